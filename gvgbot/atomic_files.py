@@ -3,7 +3,7 @@
 import contextlib
 import errno
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -20,8 +20,7 @@ def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
     try:
         for path, content in zip(aside.values(), contents.values(), strict=True):
             path.write_bytes(_encoded(content) if isinstance(content, str) else content)
-        with ThreadPoolExecutor(len(aside) or 1) as threads:  # a slow disk takes them together
-            list(threads.map(_sync, aside.values()))
+        _sync_together(aside.values())
         for path, temporary in aside.items():
             temporary.replace(path)
         sync_directory(directory)
@@ -80,6 +79,16 @@ def _encoded(text: str) -> bytes:
 def _aside(path: Path) -> Path:
     """Where a file is written before it takes its place."""
     return path.with_name(f".{path.name}.tmp")
+
+
+def _sync_together(paths: Collection[Path]) -> None:
+    """Wait until files are on the disk, which takes a slow one little longer than one of them."""
+    try:
+        with ThreadPoolExecutor(len(paths) or 1) as threads:
+            list(threads.map(_sync, paths))
+    except RuntimeError:  # no thread can be started
+        for path in paths:
+            _sync(path)
 
 
 def _sync(path: Path) -> None:

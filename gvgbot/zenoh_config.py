@@ -17,7 +17,8 @@ _COMMON: Mapping[str, object] = {
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
     "transport/unicast/open_timeout": 2000,  # ms; closing waits for it if the other end is frozen
-    "transport/unicast/accept_pending": 1000,  # connections that say nothing keep nobody else out
+    # silent ones keep others out, and 1,024 are all the files that a service may have open
+    "transport/unicast/accept_pending": 300,
     "connect/retry": {
         "period_init_ms": 100,
         "period_max_ms": 1000,

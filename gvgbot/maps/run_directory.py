@@ -109,10 +109,10 @@ class RunDirectory:
 
     def remove_blank(self) -> None:
         """Remove the directory, if nothing is in it but a list of events that is blank."""
-        self.close()
-        with contextlib.suppress(OSError):
-            (self.path / EVENTS).unlink()
-            self.path.rmdir()
+        with self._events, contextlib.suppress(OSError):
+            if self.is_blank and _is_at(self._events, self.path / EVENTS):
+                (self.path / EVENTS).unlink()
+                self.path.rmdir()
 
     @property
     def whereabouts(self) -> list[str]:

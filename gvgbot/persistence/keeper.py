@@ -187,9 +187,11 @@ class Keeper:
             if is_urgent:
                 await clock.sleep_until(next_wish)  # of a crowd all are kept at once
                 next_wish = clock.now() + KEEP_EVERY
-            self._urgent.clear()
-            if is_urgent and self._session.pipeline.errands.is_paused:
+            errands = self._session.pipeline.errands
+            is_told_to_stand = errands.is_paused and not (errands.is_carried or errands.unfit)
+            if is_urgent and is_told_to_stand:
                 await off_loop(partial(self._files.note_rest, rests=True))  # until all is written
+            self._urgent.clear()
             await off_loop(self.keeping(clock.now()))
             if not self._urgent.is_set():
                 self._wish_kept.set()

@@ -62,6 +62,17 @@ def test_a_slow_disk_takes_files_that_belong_together_at_once(
     assert contents(directory) == {"map.yaml": b"new\n", "map.png": b"new one"}
 
 
+def test_where_no_thread_can_be_started_files_are_written_all_the_same(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(thread: object) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr("threading.Thread.start", refuse)
+    write_files(directory, NEW)
+    assert contents(directory) == {"map.yaml": b"new\n", "map.png": b"new one"}
+
+
 def test_a_disk_that_does_not_take_a_file_keeps_the_old_ones(
     directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

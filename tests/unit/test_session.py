@@ -1,5 +1,6 @@
 """What is counted of a run, and what is written of it."""
 
+import contextlib
 import json
 from pathlib import Path
 
@@ -70,3 +71,19 @@ def test_the_map_is_saved_though_events_cannot_be_written(tmp_path: Path) -> Non
         with pytest.raises(GvgbotError, match=r"cannot write .*events\.jsonl"):
             session.save()
     assert {"map.geojson", "summary.json"} <= {path.name for path in directory.path.iterdir()}
+
+
+@pytest.mark.parametrize(
+    "left", ["nothing", "an event", "an event for which there was no room", "a failure"]
+)
+def test_only_where_nothing_happened_nothing_is_left_to_keep(tmp_path: Path, left: str) -> None:
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+        with contextlib.ExitStack() as stack:
+            if "no room" in left:
+                stack.enter_context(structlog.testing.capture_logs())
+                stack.enter_context(full_disk(10))
+            if "event" in left:
+                session.on_events([STUCK])
+        session.failure = left if left == "a failure" else None
+        assert session.is_blank == (left == "nothing")

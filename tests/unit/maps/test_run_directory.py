@@ -214,6 +214,15 @@ def test_a_blank_directory_goes_and_nobody_else_s_files(tmp_path: Path, others: 
     assert (tmp_path / "run").exists() == bool(others)
 
 
+def test_a_list_of_events_that_came_with_another_disk_stays(tmp_path: Path) -> None:
+    directory = RunDirectory(tmp_path / "run")
+    (tmp_path / "run").rename(tmp_path / "hidden")
+    with RunDirectory(tmp_path / "run") as other:
+        other.append_event(Recovery(1.0, "back off", "bumper"))
+    directory.remove_blank()
+    assert (tmp_path / "run" / "events.jsonl").read_text()
+
+
 def test_where_no_directory_can_be_made_for_want_of_room_that_is_the_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -361,6 +361,30 @@ def test_who_hears_that_the_robot_stands_finds_it_so_after_a_power_cut(
     run_in_virtual_time(story())
 
 
+def test_who_paused_because_it_was_carried_looks_for_its_place_after_a_restart(
+    session: Session, tmp_path: Path
+) -> None:
+    keeper, errands = Keeper(session, MissionFiles(tmp_path)), session.pipeline.errands
+    errands.is_paused = errands.is_carried = True
+
+    async def off_loop(work: Callable[[], None]) -> None:
+        await asyncio.sleep(0.05)
+        work()
+
+    async def story() -> None:
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            keeping = tasks.create_task(keeper.keep(clock, off_loop))
+            for _ in range(2):  # the second before the first is kept
+                keeper.on_event(Requested(60.0, "save", "ana", True, ""))
+                await clock.sleep_until(clock.now() + 0.03)
+            await clock.sleep_until(clock.now() + 2.0)
+            keeping.cancel()
+
+    run_in_virtual_time(story())
+    assert not found(tmp_path).memory.intent.is_paused
+
+
 def test_a_crowd_of_requests_is_kept_at_once(session: Session, tmp_path: Path) -> None:
     keeper, times = Keeper(session, MissionFiles(tmp_path)), 0
 
