@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.rigs.addresses import free_endpoint, router
-from benchmarks.rigs.programs import gvgbot
+from benchmarks.rigs.programs import gvgbot, until
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
 
@@ -88,6 +88,7 @@ def test_daemons_at_a_router_hear_each_other(tmp_path: Path) -> None:
             assert process.stdout is not None
             said = next(line for line in process.stdout if "warning" in line and "name" in line)
             assert "robot.name" in said
+        until((tmp_path / "one" / "map.geojson").exists)  # it has seen something
         two.kill()
         one.send_signal(signal.SIGTERM)
         log, _ = one.communicate(timeout=40)
