@@ -77,8 +77,8 @@ def test_daemons_at_a_router_hear_each_other(tmp_path: Path) -> None:
 
     def daemon(run: str) -> contextlib.AbstractContextManager["subprocess.Popen[str]"]:
         settings = [
-            *("robot.name=karl", "team.enabled=true", f"telemetry.connect=[{meeting}]"),
-            f"telemetry.listen=[{free_endpoint()}]",
+            *("robot.name=karl", "team.enabled=true", "twin.enabled=true", "twin.world=comb"),
+            *(f"telemetry.connect=[{meeting}]", f"telemetry.listen=[{free_endpoint()}]"),
         ]
         more = [word for setting in settings for word in ("--set", setting)]
         return gvgbot("run", *more, "--out", str(tmp_path / run), cwd=tmp_path)
