@@ -146,8 +146,7 @@ def run(
         ros2, foxglove = _ros2(config, stack, telemetry), _foxglove(config, stack)
         asked = wanted(config, os.environ, out=out, known=known, anew=anew)
         start = begin(asked, world=name, stack=stack)
-        directory = start.directory
-        session = Session(config, directory, place)
+        session = Session(config, start.directory, place)
         keeper = Keeper(session, start.files, start.saved)
         network = "off" if telemetry is None else telemetry.addresses
         _announce(session, network, resumed=start.saved is not None)
@@ -171,14 +170,19 @@ def run(
             session.failure = reason_of(failures)
             raise
         finally:
-            if session.is_blank:  # or each start without devices would leave one
-                directory.remove_blank()
-                log.info("no map saved", reason="nothing was seen")
-            else:
-                keeper.finish()
-                session.save()
-                log.info("map saved", path=str(directory.path))
+            _leave_map(session, keeper)
     return 0
+
+
+def _leave_map(session: Session, keeper: Keeper) -> None:
+    """Write what is known, if that is anything: each start without devices would leave a map."""
+    if session.is_blank:
+        session.directory.remove_blank()
+        log.info("no map saved", reason="nothing was seen")
+    else:
+        keeper.finish()
+        session.save()
+        log.info("map saved", path=str(session.directory.path))
 
 
 async def _serve(robot: Robot, signals: StopSignals) -> None:

@@ -82,7 +82,7 @@ def test_only_where_nothing_happened_nothing_is_left_to_keep(tmp_path: Path, lef
         with contextlib.ExitStack() as stack:
             if "no room" in left:
                 stack.enter_context(structlog.testing.capture_logs())
-                stack.enter_context(full_disk(10))
+                stack.enter_context(full_disk(0))
             if "event" in left:
                 session.on_events([STUCK])
         session.failure = left if left == "a failure" else None

@@ -336,10 +336,14 @@ def test_who_was_told_to_stand_stands_after_a_power_cut_though_the_disk_is_full(
 
 @pytest.mark.parametrize("takes_s", [0.0, 3.0], ids=["quick disk", "slow disk"])
 def test_who_hears_that_the_robot_stands_finds_it_so_after_a_power_cut(
-    session: Session, tmp_path: Path, takes_s: float
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, takes_s: float
 ) -> None:
-    keeper = Keeper(session, MissionFiles(tmp_path))
+    """And so does who ends the program while it waits for the disk."""
+    keeper, stands = Keeper(session, MissionFiles(tmp_path)), list[bool]()
     keeper.keeping(20.0)()
+    monkeypatch.setattr(
+        os, "fsync", lambda _: stands.append(found(tmp_path).memory.intent.is_paused)
+    )
 
     async def off_loop(work: Callable[[], None]) -> None:
         work()
@@ -359,6 +363,8 @@ def test_who_hears_that_the_robot_stands_finds_it_so_after_a_power_cut(
             keeping.cancel()
 
     run_in_virtual_time(story())
+    assert stands
+    assert all(stands)
 
 
 def test_who_paused_because_it_was_carried_looks_for_its_place_after_a_restart(
