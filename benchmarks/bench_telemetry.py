@@ -28,7 +28,6 @@ from gvgbot import client
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.keyframes import Keyframe, Step
-from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
@@ -51,6 +50,7 @@ VERTICES, BEAMS, SIDE = 200, 1081, 60.0
 STATE_HZ, MAP_HZ, SCAN_HZ, ODOMETRY_HZ = 10.0, 1.0, 40.0, 50.0
 FINE = LinkHealth(connected=True, messages=1, damaged=0, lost=0, reconnects=0, clock_offset=0.0)
 _ANGLES = np.linspace(0.0, 2.0 * math.tau, 1800)  # where it stood at each keyframe
+STEP_NOISE = np.diag([1e-4, 1e-4, 1e-4])
 LISTENER = ("-m", "benchmarks.bench_telemetry", "listen")
 
 
@@ -76,7 +76,7 @@ class Robot:
 
     def __init__(self, network: Telemetry) -> None:
         known, belief = graph()
-        self.pipeline = _mind(known, belief, "paper")  # its places follow from no motion
+        self.pipeline = _mind(known, belief)
         self.network, self.live_map = network, LiveMap(0.0)
         self.vitals = Vitals(time.perf_counter())
         self.feed = LiveFeed(network, self.pipeline, SCAN_HZ)
@@ -122,10 +122,7 @@ class Robot:
     def on_map(self) -> None:
         x, y = self.rng.uniform(0.0, SIDE, 2).tolist()
         stamp = time.perf_counter()
-        here = Pose(x, y)
-        self.pipeline.past.keyframes.append(
-            Keyframe(stamp, here, here, here, PackedScan(self.scan(stamp)))
-        )
+        self.arrive(Pose(x, y), self.scan(stamp))
         draw = self.live_map.update(self.pipeline, stamp)
         assert draw is not None
         for value, latest in draw():  # stamped when ready, so that only the way is measured
@@ -141,18 +138,22 @@ class Robot:
         """Have seen the whole map before, so that it is as large as it gets."""
         for x in np.arange(4.0, SIDE, 8.0).tolist():
             for y in np.arange(4.0, SIDE, 8.0).tolist():
-                here = Pose(x, y)
-                self.pipeline.past.keyframes.append(
-                    Keyframe(0.0, here, here, here, PackedScan(self.scan(0.0)))
-                )
+                self.arrive(Pose(x, y), self.scan(0.0))
         for at in np.linspace(0.0, 50.0, 2000).tolist():
-            there = Pose(at, at)
-            self.pipeline.past.keyframes.append(Keyframe(0.0, there, there, there, None))
+            self.arrive(Pose(at, at), None)
+
+    def arrive(self, here: Pose, scan: Scan | None) -> None:
+        """Add a keyframe, and the step that led to it."""
+        past, kept = self.pipeline.past, None if scan is None else PackedScan(scan)
+        if past.last is not None:
+            past.steps.append(Step(past.last.map_base.to(here), STEP_NOISE))
+        stamp = 0.0 if scan is None else scan.stamp
+        past.keyframes.append(Keyframe(stamp, here, here, here, kept))
 
 
-def _mind(known: GvgGraph, belief: Belief, localisation: Localisation = "full") -> Pipeline:
+def _mind(known: GvgGraph, belief: Belief) -> Pipeline:
     """A mind with a map, at its first vertex, that goes to the last."""
-    pipeline = Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177, localisation=localisation)
+    pipeline = Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177)
     pipeline.mapper.graph, pipeline.mapper.belief = known, belief
     pipeline.mission.target = HalfEdgeId(VERTICES - 1, 1)
     pipeline.mission.where.on_edge = HalfEdgeId(0, 0)
@@ -222,7 +223,6 @@ def redrawing() -> tuple[float, float]:
     way = [Pose(20.0 * math.sin(a), 20.0 * (1.0 - math.cos(a)), a) for a in _ANGLES.tolist()]
     pipeline, rng = _mind(GvgGraph(), Belief()), np.random.default_rng(1)
     far = [Pose(1.01 * pose.x, 1.01 * pose.y, pose.theta) for pose in way]
-    noise = np.diag([1e-4, 1e-4, 1e-4])
     step = math.radians(270.0) / (BEAMS - 1)
     for i, (true, believed) in enumerate(zip(way, far, strict=True)):
         seen = Scan(0.1 * i, rng.uniform(2.0, 12.0, BEAMS), -2.35, step, 0.1, 30.0)
@@ -230,7 +230,7 @@ def redrawing() -> tuple[float, float]:
             0.1 * i, believed, believed, believed, None if i % 3 else PackedScan(seen)
         )
         pipeline.past.keyframes.append(keyframe)
-        pipeline.past.steps.append(Step(true.to(way[min(i + 1, len(way) - 1)]), noise))
+        pipeline.past.steps.append(Step(true.to(way[min(i + 1, len(way) - 1)]), STEP_NOISE))
     live_map, begin = LiveMap(0.0), time.perf_counter()
     draw = live_map.update(pipeline, 1.0)
     held, used = time.perf_counter() - begin, cpu()
