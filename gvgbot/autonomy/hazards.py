@@ -42,7 +42,7 @@ class Hazards:
 
     def __init__(self, config: HazardConfig) -> None:
         self._config = config
-        self._all: list[Hazard] = []
+        self.felt: list[Hazard] = []
         self.virtual_walls = np.empty((0, 2))  # points of those in reach, local frame
 
     def add(
@@ -60,29 +60,40 @@ class Hazards:
         """
         self.forget(travelled)
         hazard = Hazard(_rim(local_base, bearings, radius + _BEYOND_M), travelled, lasting)
-        away = [float(np.hypot(*(other.centre - hazard.centre))) for other in self._all]
-        for other, metres in zip(self._all, away, strict=True):
+        away = [float(np.hypot(*(other.centre - hazard.centre))) for other in self.felt]
+        for other, metres in zip(self.felt, away, strict=True):
             if metres < self._config.same_m:
                 other.lasting = hazard.lasting = True
-        self._all.append(hazard)
+        self.felt.append(hazard)
         hits = 1 + sum(metres < self._config.blocking_m for metres in away)
         return hits >= self._config.blocking_hits
 
+    def take_over(self, other: "Hazards", other_own: Pose, metres: float) -> None:
+        """Go on in another's local frame, which sees this one's at a pose, with what it has felt.
+
+        Since it began to count so many metres had been driven.
+        """
+        for hazard in self.felt:
+            hazard.points = other_own.transform(hazard.points)
+        for hazard in other.felt:
+            hazard.travelled += metres
+        self.felt += other.felt
+
     def forget(self, travelled: float) -> None:
         """Let go what was felt too long ago, in metres driven."""
-        self._all = [
-            h for h in self._all if h.lasting or travelled - h.travelled < self._config.memory_m
+        self.felt = [
+            h for h in self.felt if h.lasting or travelled - h.travelled < self._config.memory_m
         ]
 
     @property
     def points(self) -> Array:
         """All of them (N, 2), local frame, virtual walls as well."""
-        return np.concatenate([*(h.points for h in self._all), self.virtual_walls])
+        return np.concatenate([*(h.points for h in self.felt), self.virtual_walls])
 
     @property
     def doubtful(self) -> Array:
         """Those that were felt only once (N, 2), local frame."""
-        once = (h.points for h in self._all if not h.lasting)
+        once = (h.points for h in self.felt if not h.lasting)
         return np.concatenate([np.empty((0, 2)), *once])
 
 

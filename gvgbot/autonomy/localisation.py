@@ -109,6 +109,12 @@ class LocalMaps:
         if self._walls is None:
             self._walls = self._drawn()
 
+    def count_on(self, metres: float) -> None:
+        """Take what was driven as so much more: the counting began elsewhere."""
+        self._teach_far()
+        self.near.count_on(metres)
+        self._far.count_on(metres)
+
     def _teach_far(self) -> None:
         if self._due is not None:
             self._far.insert(*self._due)

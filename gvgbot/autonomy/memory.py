@@ -160,7 +160,7 @@ def remember(pipeline: Pipeline) -> Memory:
             calibration.told,
             calibration.shared,
         ),
-        hazards=pipeline._hazards._all,
+        hazards=pipeline._hazards.felt,
         newcomers=pipeline.traffic.newcomers._all,
         lasting=past.lasting,
         passed=pipeline.traffic.passed,
@@ -254,7 +254,7 @@ def recall(pipeline: Pipeline, memory: Memory, grown: list[Growth]) -> None:
     if len(memory.odds.noises) == len(calibration.noise):  # else it is of an older version
         calibration.noise, calibration.told = memory.odds.noises, memory.odds.told_of
     calibration.shared = memory.odds.common
-    pipeline._hazards._all = list(memory.hazards)
+    pipeline._hazards.felt = list(memory.hazards)
     pipeline.traffic.newcomers._all = list(memory.newcomers)
     pipeline.traffic.passed, pipeline.traffic.lasting = memory.passed, []
     past = pipeline.past

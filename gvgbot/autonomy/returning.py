@@ -224,10 +224,9 @@ class ReturningPipeline(Pipeline):
         )
         map_base = self.mapper.belief.map_base
         map_local = map_base.compose(found.local_base.inverse())
-        self._move_hazards(seeker, map_local.to(map_before))
-        older = self.past.travelled - seeker.past.travelled
-        for local_map in (seeker.tracker.maps.near, seeker.tracker.maps._far):
-            local_map._seen_at += np.float32(older)
+        before = self.past.travelled - seeker.past.travelled
+        self._hazards.take_over(seeker._hazards, map_local.to(map_before), before)
+        seeker.tracker.maps.count_on(before)
         self.tracker.take_over(seeker.tracker)
         self.gvg, self._reflexes = seeker.gvg, seeker._reflexes
         self.traffic.newcomers = seeker.traffic.newcomers
@@ -237,14 +236,6 @@ class ReturningPipeline(Pipeline):
         self.past.with_scan = None
         self._look_now = self._is_back = True
         self._end_seeking(seeker)
-
-    def _move_hazards(self, seeker: Pipeline, turn: Pose) -> None:
-        """Take what was felt into the new local frame, which sees the old one at `turn`."""
-        for hazard in self._hazards._all:
-            hazard.points = turn.transform(hazard.points)
-        for hazard in seeker._hazards._all:
-            hazard.travelled += self.past.travelled - seeker.past.travelled
-        self._hazards._all += seeker._hazards._all
 
 
 def _given_up(opinion: Opinion) -> str:

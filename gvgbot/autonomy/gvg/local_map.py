@@ -218,6 +218,10 @@ class LocalMap:
         disc = self._disc(centre, radius)
         self._free[disc], self._seen_at[disc] = True, travelled
 
+    def count_on(self, metres: float) -> None:
+        """Take what was driven as so much more: the counting began elsewhere."""
+        self._seen_at += np.float32(metres)
+
     def _disc(self, centre: Array, radius: float) -> tuple[Index, Index]:
         """Rows and columns of the cells whose middles lie in a disc, local frame."""
         reach = math.ceil(radius / self._cell)

@@ -64,3 +64,18 @@ def test_three_hits_within_a_metre_block_the_way() -> None:
     assert not felt(hazards, 0.5, 1.0)
     assert not felt(hazards, 5.0, 6.0)  # elsewhere
     assert felt(hazards, 0.9, 10.0)
+
+
+def test_who_goes_on_in_another_frame_keeps_both_ones_hazards() -> None:
+    """The other one began to count after 100 m, at (3, 0) in the own frame, turned to the left."""
+    own, other = Hazards(HazardConfig()), Hazards(HazardConfig())
+    felt(own, 0.0, 95.0)
+    felt(other, 5.0, 2.0)
+    (before,), (theirs,) = own.felt, other.felt
+    there, here = before.points.copy(), theirs.points.copy()
+    own.take_over(other, Pose(3.0, 0.0, math.pi / 2).inverse(), 100.0)
+    x, y = there.T
+    np.testing.assert_allclose(own.felt[0].points, np.stack([y, 3.0 - x], axis=1), atol=1e-12)
+    np.testing.assert_allclose(own.felt[1].points, here)
+    own.forget(101.0 + MEMORY)  # 95 is too long ago, 102 is not
+    assert own.felt == [theirs]

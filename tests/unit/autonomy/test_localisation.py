@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -331,3 +332,19 @@ def test_a_thin_wall_seen_from_behind_is_not_taken_for_the_face_seen_before() ->
         local.insert(scan, believed, 0.3 * len(errors))
         errors.append(abs(believed.y - here.y))
     assert max(errors) < 0.5 * thin
+
+
+def test_what_was_learnt_last_is_not_old_either_when_it_counts_on() -> None:
+    """Both maps forget by metres driven, and the far one learns a scan late."""
+    local, seen = maps(), room(np.random.default_rng(1), 0.0)
+    blind = replace(seen, ranges=np.full(len(BEARINGS), np.nan))
+    local.insert(seen, Pose(), 3.0)
+    local.count_on(1000.0)
+    local.insert(blind, Pose(), 1003.1)
+    local.catch_up()
+    near, far = len(local.near.points()), len(local._far.points())
+    fresh = maps()
+    fresh.insert(seen, Pose(), 3.0)
+    fresh.catch_up()
+    assert (near, far) == (len(fresh.near.points()), len(fresh._far.points()))
+    assert min(near, far) > 100

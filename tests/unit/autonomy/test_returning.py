@@ -284,13 +284,13 @@ def test_what_was_seen_and_felt_before_and_meanwhile_is_where_it_was_when_the_pl
     robot._hazards.add(Pose(2.0, 1.0, 2.0), (0.0,), 0.2, 0.0, lasting=True)
     seeker._hazards.add(Pose(0.5), (0.0,), 0.2, 2.0, lasting=False)
     before = robot.mapper.belief.map_base.compose(last.local_base.inverse())
-    stairs = before.transform(robot._hazards._all[-1].points)
-    post = seeker._hazards._all[0].points.copy()
+    stairs = before.transform(robot._hazards.felt[-1].points)
+    post = seeker._hazards.felt[0].points.copy()
     robot._arrive(seeker, Pose(1.0, 0.5, 0.3))
     found = robot.past.last
     assert found is not None
     now = robot.mapper.belief.map_base.compose(found.local_base.inverse())
-    *_, first, second = robot._hazards._all
+    *_, first, second = robot._hazards.felt
     assert now.transform(first.points) == pytest.approx(stairs)
     assert second.points == pytest.approx(post)
     assert robot.past.travelled - second.travelled == pytest.approx(1.0)
