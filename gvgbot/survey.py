@@ -12,7 +12,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Array, Pose, anchored, sampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps, is_wall
-from gvgbot.maps.hits import Scans, barred, hits
+from gvgbot.maps.hits import Scans, barred, stood_s
 from gvgbot.maps.hollows import bodies, hollows
 from gvgbot.maps.in_sight import are_nearer_to
 from gvgbot.maps.narrows import narrows
@@ -158,9 +158,9 @@ def _at_ends(pipeline: Pipeline) -> Array:
 
 
 def _may_go(places: Array, scans: Scans, pipeline: Pipeline) -> Array:
-    """Those bodies (M, 2) of some (N, 2) that were not in sight for so long that they stay."""
+    """Those bodies (M, 2) of some (N, 2) that have not stood for so long that they stay."""
     lasting_s = pipeline.traffic.newcomers.longest_patience
-    return np.asarray(places[hits(scans, places, _BODY_M).seconds < lasting_s])
+    return np.asarray(places[stood_s(scans, places, _BODY_M) < lasting_s])
 
 
 def _barred(

@@ -1,13 +1,14 @@
-"""Hits of scans: how often, and for how long, there was something to be seen at places."""
+"""Hits of scans: how often something was seen at places, and for how long it has stood there."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gvgbot.autonomy.on_bodies import is_seen_through
 from gvgbot.geometry import Array, Pose, resampled
+from gvgbot.hal.messages import Scan
 from gvgbot.hal.packed_scan import AnyScan
 from gvgbot.maps.gaps import is_wall
 from gvgbot.maps.occupancy import OccupancyGrid
@@ -16,34 +17,46 @@ _STEP_M = 0.1  # between points of a way
 _ON_M = 0.1  # nearer to a way than any wall beside it, a wall is on it
 _DRIVEN_M = 0.3  # so near to where it has been, the robot may drive
 _LOOKS = 3  # that hit a wall at one place; people who pass by are hit there once or twice
-_IN_SIGHT_S = 5.0  # from look to look; later, somebody else may stand there
+_CORE_M = 0.1  # of somebody: who sees through it sees that he has gone
 
 Scans = Sequence[tuple[Pose, AnyScan]]  # where each was taken (map_base)
 
 
-class Hits(NamedTuple):
-    """How many scans hit each of some places (N,), and for how long, s, it was in sight of them."""
-
-    looks: NDArray[np.int64]
-    seconds: Array
-
-
-def hits(scans: Scans, places: Array, within_m: float) -> Hits:
-    """The hits near places (N, 2), m, map frame: each counts for the nearest one.
-
-    Scans come in the order of their stamps.
-    """
-    looks = np.zeros(len(places) + 1, np.int64)  # the last one for what is farther off
-    seconds, latest = np.zeros(len(looks)), np.full(len(looks), -np.inf)
-    tree = cKDTree(places)
-    for map_base, scan in scans if len(places) else ():
-        ends = map_base.compose(scan.base_laser).transform(scan.unpacked().ends)
-        found = np.unique(tree.query(ends, distance_upper_bound=within_m)[1])
-        since = scan.stamp - latest[found]
+def hits(scans: Scans, places: Array, within_m: float) -> NDArray[np.int64]:
+    """How many scans hit something near places (N, 2), m, map frame; each hit is the nearest's."""
+    looks = np.zeros(len(places), np.int64)
+    for _, _, found in _looks(scans, places, within_m):
         looks[found] += 1
-        seconds[found] += np.where((since > 0.0) & (since < _IN_SIGHT_S), since, 0.0)
-        latest[found] = scan.stamp
-    return Hits(looks[:-1], seconds[:-1])
+    return looks
+
+
+def stood_s(scans: Scans, places: Array, within_m: float) -> Array:
+    """For how long (N,), s, something has stood near places (N, 2), m, map frame.
+
+    From the first scan that hit it to the last one, also where nobody looked in between; but not
+    if a scan sees through the place: then it was somebody else before. Scans come in the order of
+    their stamps.
+    """
+    first, last = np.full(len(places), np.nan), np.full(len(places), np.nan)
+    for map_base, scan, found in _looks(scans, places, within_m):
+        for place in np.flatnonzero(np.isfinite(first)):
+            if is_seen_through(scan, map_base, (places[place], _CORE_M)):
+                first[place] = last[place] = np.nan
+        first[found] = np.where(np.isnan(first[found]), scan.stamp, first[found])
+        last[found] = scan.stamp
+    return np.asarray(np.nan_to_num(last - first))
+
+
+def _looks(
+    scans: Scans, places: Array, within_m: float
+) -> Iterator[tuple[Pose, Scan, NDArray[np.intp]]]:
+    """All scans, with where they were taken and which of the places (N, 2) they hit."""
+    tree = cKDTree(places)
+    for map_base, packed in scans if len(places) else ():
+        scan = packed.unpacked()
+        ends = map_base.compose(scan.base_laser).transform(scan.ends)
+        near = np.asarray(tree.query(ends, distance_upper_bound=within_m)[1])
+        yield map_base, scan, np.unique(near[near < len(places)])
 
 
 def barred(
@@ -60,5 +73,5 @@ def barred(
     walls = grid.middles(is_wall(grid.cells))
     is_left = cKDTree(driven).query(points)[0] > _DRIVEN_M
     is_left &= cKDTree(walls).query(points)[0] > _ON_M
-    is_hit = hits(scans, points[is_left], _ON_M).looks >= _LOOKS
+    is_hit = hits(scans, points[is_left], _ON_M) >= _LOOKS
     return np.isin(np.arange(len(lines)), number[is_left][is_hit])

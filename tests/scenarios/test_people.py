@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import dropwhile, pairwise, takewhile
 
 import numpy as np
 import pytest
@@ -272,8 +272,9 @@ def test_who_stands_in_the_middle_of_a_room_is_driven_round_but_once() -> None:
             await run.sleep(0.1)
         before = len(run.truth)
         await run.sleep(70.0)
-        there = [(p.x, p.y) for p in run.truth[before:] if p.y < 5.2]
-        driven.append(sum(math.dist(*pair) for pair in pairwise(there)))
+        inside = dropwhile(lambda p: p.y > 5.2, run.truth[before:])
+        stay = [(p.x, p.y) for p in takewhile(lambda p: p.y < 5.2, inside)]
+        driven.append(sum(math.dist(*pair) for pair in pairwise(stay)))
         run.put_person(*FAR_AWAY)
 
     twin = TwinConfig(seed=3, laser=HokuyoTwinConfig(model="URG-04LX"))
@@ -281,4 +282,4 @@ def test_who_stands_in_the_middle_of_a_room_is_driven_round_but_once() -> None:
     run = play(world, Pose(-1.0, 10.6, 0.1), story=story, with_person=True, twin=twin)
     assert run.outcome == "explored", run.pipeline.mission.reason
     assert run.contacts == 0
-    assert driven[0] < 1.5 * math.tau * 1.8
+    assert 0.5 * math.tau * 1.8 < driven[0] < 1.5 * math.tau * 1.8

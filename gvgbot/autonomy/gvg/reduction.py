@@ -24,7 +24,7 @@ from gvgbot.geometry import Array
 from gvgbot.ranges import Range
 
 _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
-_REACH_HYSTERESIS = 1.12
+_REACH_HYSTERESIS = 1.1
 _SEEN_SHARE = 0.8  # of the laser's range: walls farther off may lack
 _CORNER_SHARE = 0.7  # of the map's reach: a corner is sqrt(2) times as far as its walls
 _SPECK = 4.0  # so many of the shortest edges around open space are no way round it
@@ -60,7 +60,7 @@ class KnownVertices:
 class ReductionConfig:
     """What is worth being a vertex."""
 
-    min_reach: Annotated[float, Range(1.45, 4.0)] = 1.7  # shorter dangling branches are corners
+    min_reach: Annotated[float, Range(1.45, 4.0)] = 1.6  # shorter dangling branches are corners
     merge_m: Annotated[float, Range(0.0, 2.0)] = 0.6  # meetpoints closer than this are one
     roughness_m: Annotated[float, Range(0.0, 0.2)] = (
         0.03  # unevenness of a flat wall, noise included

@@ -7,7 +7,7 @@ import pytest
 
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose
-from gvgbot.maps.hits import Scans, barred, hits
+from gvgbot.maps.hits import Scans, barred, hits, stood_s
 from gvgbot.maps.occupancy import occupancy_grid
 from tests.unit.autonomy.sights import carved, sweep
 
@@ -44,19 +44,26 @@ def test_without_ways_none_is_barred() -> None:
     assert len(barred(seen_from(0.0), [], grid, NOWHERE)) == 0
 
 
-def test_it_is_told_how_often_and_how_long_a_post_was_in_sight() -> None:
-    """When nobody has looked for more than five seconds, it may be another one."""
-    scans = [
-        (pose, replace(sweep(world, pose), stamp=stamp))
-        for world, pose, stamp in (
-            (WALLED, Pose(0.0), 1.0),
-            (POST, Pose(0.0), 2.0),
-            (POST, Pose(0.5), 5.0),
-            (POST, Pose(1.0), 9.0),
-            (WALLED, Pose(1.0), 10.0),
-            (POST, Pose(1.0), 30.0),
-        )
-    ]
-    seen = hits(scans, np.array([[2.0, 0.5], [-2.0, 0.0]]), 0.3)
-    assert seen.looks.tolist() == [4, 0]
-    assert seen.seconds.tolist() == [7.0, 0.0]
+def seen_at(*looks: tuple[World, float, float]) -> Scans:
+    """Scans of worlds from points of the middle line, x, m, at their stamps, s."""
+    return [(Pose(x), replace(sweep(world, Pose(x)), stamp=stamp)) for world, x, stamp in looks]
+
+
+PLACES = np.array([[2.0, 0.5], [-2.0, 0.0]])  # of the post, and of nothing
+CAME = (WALLED, 0.0, 1.0), (POST, 0.0, 2.0), (POST, 0.5, 5.0), (POST, 1.0, 9.0)
+
+
+def test_it_is_told_how_many_scans_hit_a_post() -> None:
+    assert hits(seen_at(*CAME), PLACES, 0.3).tolist() == [3, 0]
+
+
+def test_who_is_found_where_he_stood_has_stood_there_all_the_time() -> None:
+    assert stood_s(seen_at(*CAME), PLACES, 0.3).tolist() == [7.0, 0.0]
+    again = (POST, 0.5, 130.0)
+    assert stood_s(seen_at(*CAME, again), PLACES, 0.3).tolist() == [128.0, 0.0]
+
+
+def test_who_stands_where_somebody_has_gone_has_not_stood_there_before() -> None:
+    gone, other = (WALLED, 1.0, 60.0), ((POST, 0.5, 130.0), (POST, 0.0, 140.0))
+    assert stood_s(seen_at(*CAME, gone, *other), PLACES, 0.3).tolist() == [10.0, 0.0]
+    assert stood_s(seen_at(*CAME, gone), PLACES, 0.3).tolist() == [0.0, 0.0]
