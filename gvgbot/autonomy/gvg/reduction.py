@@ -24,7 +24,8 @@ from gvgbot.geometry import Array
 from gvgbot.ranges import Range
 
 _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
-_REACH_HYSTERESIS = 1.1
+_REACH_HYSTERESIS = 1.12
+_END_REACH = 1.6  # of a niche that an edge ends in, beside corners; one in a right angle has 1.41
 _SEEN_SHARE = 0.8  # of the laser's range: walls farther off may lack
 _CORNER_SHARE = 0.7  # of the map's reach: a corner is sqrt(2) times as far as its walls
 _SPECK = 4.0  # so many of the shortest edges around open space are no way round it
@@ -60,7 +61,7 @@ class KnownVertices:
 class ReductionConfig:
     """What is worth being a vertex."""
 
-    min_reach: Annotated[float, Range(1.45, 4.0)] = 1.6  # shorter dangling branches are corners
+    min_reach: Annotated[float, Range(1.45, 4.0)] = 1.7  # shorter dangling branches are corners
     merge_m: Annotated[float, Range(0.0, 2.0)] = 0.6  # meetpoints closer than this are one
     roughness_m: Annotated[float, Range(0.0, 0.2)] = (
         0.03  # unevenness of a flat wall, noise included
@@ -90,7 +91,10 @@ def reduce_graph(
 
 
 def _prune(draft: Draft, min_reach: float, endpoints: Array) -> None:
-    """Drop corner branches in rounds: a dead end keeps the vertex that both its corners hang on."""
+    """Drop corner branches in rounds: a dead end keeps the vertex that both its corners hang on.
+
+    Or it goes on into the deepest of them, if that is rather a niche.
+    """
     while True:
         doomed: dict[int, list[tuple[int, int]]] = {}  # leaves and their chains, by base
         for node, ends in draft.ends.items():
@@ -106,11 +110,24 @@ def _prune(draft: Draft, min_reach: float, endpoints: Array) -> None:
         least = min((draft.clearance[fork] for fork in forks), default=math.inf)
         ready = [base for base in doomed if draft.clearance[base] <= least]
         for base in ready:
-            for node, key in doomed[base]:
+            for node, key in _corners(draft, base, doomed[base], endpoints):
                 draft.drop_leaf(node, key, base)
         for base in ready:
             if base in draft.ends and len(draft.ends[base]) == 2 and not draft.open(base):
                 draft.splice(base)
+
+
+def _corners(
+    draft: Draft, base: int, doomed: list[tuple[int, int]], endpoints: Array
+) -> list[tuple[int, int]]:
+    """Those of the doomed leaves of a base that go: all but a niche that its only edge ends in."""
+    if draft.degree(base) - len(doomed) > 1:
+        return doomed
+    deepest = max(doomed, key=lambda leaf: draft.reach(leaf[0])[0])
+    share = draft.reach(deepest[0])[0] / _END_REACH
+    if _is_corner(share, draft.position[deepest[0]], draft.position[base], endpoints):
+        return doomed
+    return [leaf for leaf in doomed if leaf != deepest]
 
 
 def _forks(draft: Draft, base: int, doomed: dict[int, list[tuple[int, int]]]) -> Iterator[int]:
