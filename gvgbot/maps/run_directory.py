@@ -68,6 +68,7 @@ class RunDirectory:
 
     def write(self, contents: Mapping[str, bytes | str]) -> None:
         """Replace these files together; if that fails (GvgbotError), the old ones stand."""
+        self._make_again()
         write_files(self.path, contents)
 
     def write_summary(self, summary: Mapping[str, object]) -> None:
@@ -83,6 +84,7 @@ class RunDirectory:
         Raises TypeError if the event is no dataclass, GvgbotError if the line cannot be written.
         """
         line = json.dumps(record_of(event), ensure_ascii=False, allow_nan=False) + "\n"
+        self._make_again()
         try:
             if not _is_at(self._events, self.path / EVENTS):
                 before, self._events = self._events, _list_of_events(self.path / EVENTS)
@@ -92,6 +94,11 @@ class RunDirectory:
                 self._turn_over()
         except OSError as error:
             raise GvgbotError(f"cannot write {self.path / EVENTS}: {error.strerror}") from error
+
+    def _make_again(self) -> None:
+        """Make the directory, if somebody has removed it; the one around it goes with its disk."""
+        with contextlib.suppress(OSError):  # whoever writes there tells
+            self.path.mkdir()
 
     def _turn_over(self) -> None:
         """Begin a new list of events; go on with the old one if that is not possible."""

@@ -157,18 +157,18 @@ def test_what_a_power_cut_has_left_of_an_event_is_cut_off(tmp_path: Path, rest: 
 
 def test_events_go_on_on_a_disk_that_was_out_for_a_while(tmp_path: Path) -> None:
     disk, pulled_out = tmp_path / "disk", tmp_path / "elsewhere"
-    with RunDirectory(disk) as run:
+    with RunDirectory(disk / "run") as run:
         run.append_event(LoopClosed(1.0, 1, 0.0))
         disk.rename(pulled_out)
         with pytest.raises(GvgbotError, match="No such file"):
             run.append_event(LoopClosed(2.0, 2, 0.0))
         shutil.copytree(pulled_out, disk)
-        with (disk / "events.jsonl").open("ab") as events:
+        with (disk / "run" / "events.jsonl").open("ab") as events:
             events.write(b'{"event": "loop_cl')
         run.append_event(LoopClosed(2.0, 2, 0.0))
-    lines = (disk / "events.jsonl").read_text().splitlines()
+    lines = (disk / "run" / "events.jsonl").read_text().splitlines()
     assert [json.loads(line)["stamp"] for line in lines] == [1.0, 2.0]
-    assert len((pulled_out / "events.jsonl").read_text().splitlines()) == 1
+    assert len((pulled_out / "run" / "events.jsonl").read_text().splitlines()) == 1
 
 
 def test_a_list_that_was_removed_begins_anew(tmp_path: Path) -> None:
@@ -212,6 +212,25 @@ def test_a_blank_directory_goes_and_nobody_else_s_files(tmp_path: Path, others: 
     directory.remove_blank()
     assert {path.name for path in tmp_path.glob("run/*")} == others
     assert (tmp_path / "run").exists() == bool(others)
+
+
+def test_a_directory_that_somebody_removes_is_made_again(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path / "runs" / "office-1") as directory:
+        directory.append_event(LoopClosed(1.0, 3, 0.5))
+        shutil.rmtree(directory.path)
+        directory.append_event(LoopClosed(2.0, 3, 0.5))
+        assert names(directory.path) == {"events.jsonl"}
+        shutil.rmtree(directory.path)
+        directory.write({"map.geojson": "{}"})
+        assert names(directory.path) == {"map.geojson"}
+
+
+def test_a_directory_is_not_made_where_its_disk_has_gone(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path / "disk" / "runs" / "office-1") as directory:
+        shutil.rmtree(tmp_path / "disk" / "runs")
+        with pytest.raises(GvgbotError, match="No such file"):
+            directory.write({"map.geojson": "{}"})
+        assert names(tmp_path / "disk") == set()
 
 
 def test_a_list_of_events_that_came_with_another_disk_stays(tmp_path: Path) -> None:
