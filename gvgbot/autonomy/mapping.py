@@ -8,6 +8,7 @@ from gvgbot.autonomy.association import is_crowded, pair_tracked, sightings_of
 from gvgbot.autonomy.candidates import Candidates, Mistake
 from gvgbot.autonomy.events import Event, LoopClosed, VertexMoved
 from gvgbot.autonomy.evidence import Evidence, MappingConfig
+from gvgbot.autonomy.gvg.between import between
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalNode
 from gvgbot.autonomy.map_edits import MapEdits
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
@@ -24,6 +25,7 @@ from gvgbot.autonomy.views import Correspondence, Observation, View, touches
 from gvgbot.geometry import Array, Pose
 
 _ODD = 9.0  # squared Mahalanobis distance, 2 degrees of freedom, of a sight that counts less
+_WALLS, _ROOMIER_M = 3, 0.05  # around a meetpoint or an endpoint; by which one place beats another
 _ELSEWHERE, _IN_A_ROW = 18.0, 3  # the same of sights that show, so many, that it stands elsewhere
 _TOGETHER = 1.6  # times the sigma of each, as the sights of one visit err together
 _MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
@@ -233,7 +235,8 @@ class Mapper(MapEdits):
         r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, own)
         off = ekf.mahalanobis(r, S)
         if vertex.settled and away < self._config.trust_m:
-            vertex.elsewhere = vertex.elsewhere + 1 if off > _ELSEWHERE else 0
+            is_elsewhere = off > _ELSEWHERE and not self._is_still_there(view, vertex)
+            vertex.elsewhere = vertex.elsewhere + 1 if is_elsewhere else 0
         if vertex.elsewhere >= _IN_A_ROW:
             self._place_anew(view, vertex)
             return
@@ -243,6 +246,16 @@ class Mapper(MapEdits):
         self.redraw(vertex, before)
         R = odd * _TOGETHER**2 * own
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
+
+    def _is_still_there(self, view: View, vertex: Vertex) -> bool:
+        """Whether it lies between three walls as before, and has more room than where it is seen.
+
+        What has been forgotten of the floor around it moves the GVG towards what is known.
+        """
+        place = self.belief.map_vertex(vertex.id).position
+        before = between(view.local_map, self.map_in_local(view.local_base).transform(place))
+        now = between(view.local_map, vertex.local.position)
+        return before.walls >= _WALLS and before.clearance > now.clearance + _ROOMIER_M
 
     def _place_anew(self, view: View, vertex: Vertex) -> None:
         """Believe a vertex where it is seen now, and forget what was seen of it before.

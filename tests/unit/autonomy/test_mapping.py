@@ -192,6 +192,15 @@ def test_a_vertex_beside_which_somebody_stood_is_placed_where_it_is_seen_later()
         np.testing.assert_allclose(ends, [start.position, end.position], atol=0.06)
 
 
+def test_a_vertex_between_the_walls_it_was_found_between_stays() -> None:
+    """Part of the floor around it has been forgotten, and the GVG of the rest passes by it."""
+    room = looked(carved([(1.8, -1.2, 4.2, 1.2)]), [Pose(3.0, 0.0)])
+    seen = Seen().look(TEE, 30)
+    aside = drawn(TEE_POINTS | {2: (3.5, 0.0)}, TEE_LINES, unseen=UNSEEN)
+    seen.look(aside, 60, local_map=room)
+    assert of_type(seen.events, VertexMoved) == []
+
+
 def test_what_lies_on_an_edge_nearer_than_its_walls_lies_on_a_way() -> None:
     """The edge goes from (3, 0) to (3, -4), a metre away from its walls."""
     mapper = Seen().look(TEE, 30).mapper

@@ -1,0 +1,58 @@
+"""What walls places lie between: expected by geometry."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.gvg.between import between
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.drivers.world import World
+from gvgbot.geometry import Pose
+from gvgbot.worlds.canvas import Canvas
+from tests.unit.autonomy.sights import carved, looked
+
+CORRIDOR = (-6.0, -1.0, 6.0, 1.0)
+TEE = carved(
+    [CORRIDOR, (-1.0, -6.0, 1.0, 1.0)]
+)  # from (0, -0.25) both corners are as far as the wall
+ROUND = 2.0
+
+
+def disc() -> World:
+    canvas = Canvas(6.0, 6.0, 0.02)
+    canvas.carve_disc(3.0, 3.0, ROUND)
+    return replace(canvas.world("disc"), origin=(-3.0, -3.0))
+
+
+@pytest.mark.parametrize(
+    ("world", "place", "clearance", "walls"),
+    [
+        (carved([CORRIDOR]), (0.0, 0.0), 1.0, 2),
+        (carved([CORRIDOR]), (0.0, 0.4), 0.6, 1),
+        (carved([CORRIDOR]), (5.0, 0.0), 1.0, 3),  # where it ends
+        (carved([(-6.0, -0.4, 6.0, 0.4)]), (0.0, 0.0), 0.4, 2),
+        (TEE, (0.0, -0.25), 1.25, 3),
+        (TEE, (0.0, -3.0), 1.0, 2),
+        (TEE, (0.0, 0.4), 0.6, 1),
+        (carved([(-2.0, -2.0, 2.0, 2.0)]), (0.0, 0.0), 2.0, 4),
+        (carved([(-2.0, -2.0, 2.0, 2.0)]), (-1.0, -1.0), 1.0, 2),  # on the way into a corner
+    ],
+)
+def test_it_lies_between_the_walls_that_are_equally_near(
+    world: World, place: tuple[float, float], clearance: float, walls: int
+) -> None:
+    path = [Pose(x, 0.0) for x in np.arange(-1.5, 1.6, 0.5).tolist()]
+    found = between(looked(world, path), np.array(place))
+    assert found.clearance == pytest.approx(clearance, abs=0.03)
+    assert found.walls == walls
+
+
+def test_a_round_wall_is_on_all_sides() -> None:
+    local_map = looked(disc(), [Pose(0.0, 0.0, math.pi / 4)])
+    assert between(local_map, np.zeros(2)).walls >= 3
+
+
+def test_where_nothing_is_seen_there_are_no_walls() -> None:
+    assert between(LocalMap(LocalMapConfig()), np.zeros(2)) == (math.inf, 0)
