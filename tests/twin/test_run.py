@@ -196,17 +196,17 @@ def test_a_map_that_could_not_be_saved_is_saved_as_soon_as_that_is_possible(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     path = daemon.session.directory.path
-    away = path.with_name("unplugged")
+    disk, away = path.parent, path.parent.with_name("unplugged")
     reasons: list[str] = []
 
     async def story(clock: Clock) -> None:
         await clock.sleep_until(4.0)
-        path.rename(away)
+        disk.rename(away)
         monkeypatch.setattr(run_directory, "_append", full)
         answer = await daemon.network.ask("stop")
         assert "map not saved" in answer.text
         await clock.sleep_until(4.0 + SAVE_EVERY + 2.0)  # it has tried once more
-        away.rename(path)
+        away.rename(disk)
         monkeypatch.undo()
         await clock.sleep_until(4.0 + 2 * SAVE_EVERY + 2.0)
         reasons.append(json.loads((path / "summary.json").read_text())["reason"])
