@@ -1,5 +1,6 @@
 """Hits of scans: how often something was seen at places, and for how long it has stood there."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -34,17 +35,29 @@ def stood_s(scans: Scans, places: Array, within_m: float) -> Array:
     """For how long (N,), s, something has stood near places (N, 2), m, map frame.
 
     From the first scan that hit it to the last one, also where nobody looked in between; but not
-    if a scan sees through the place: then it was somebody else before. Scans come in the order of
-    their stamps.
+    if a scan sees through the place: then it was somebody else before. Scans come as they were
+    taken; where stamps go back the clock began anew, and nobody knows how long that took.
     """
     first, last = np.full(len(places), np.nan), np.full(len(places), np.nan)
+    before = -np.inf
     for map_base, scan, found in _looks(scans, places, within_m):
-        for place in np.flatnonzero(np.isfinite(first)):
+        if scan.stamp < before:
+            first[:] = last[:] = np.nan
+        before = scan.stamp
+        for place in np.flatnonzero(np.isfinite(first) & _in_view(scan, map_base, places)):
             if is_seen_through(scan, map_base, (places[place], _CORE_M)):
                 first[place] = last[place] = np.nan
         first[found] = np.where(np.isnan(first[found]), scan.stamp, first[found])
         last[found] = scan.stamp
     return np.asarray(np.nan_to_num(last - first))
+
+
+def _in_view(scan: Scan, map_base: Pose, places: Array) -> NDArray[np.bool_]:
+    """Whether the beam towards each of the places (N, 2), map frame, gets as far as that."""
+    x, y = map_base.compose(scan.base_laser).inverse().transform(places).T
+    beam = np.round((np.arctan2(y, x) - scan.angle_min) % math.tau / scan.angle_increment)
+    told = scan.ranges[np.minimum(beam.astype(np.intp), len(scan.ranges) - 1)]
+    return np.asarray((beam < len(scan.ranges)) & (told > np.hypot(x, y)))
 
 
 def _looks(

@@ -67,3 +67,8 @@ def test_who_stands_where_somebody_has_gone_has_not_stood_there_before() -> None
     gone, other = (WALLED, 1.0, 60.0), ((POST, 0.5, 130.0), (POST, 0.0, 140.0))
     assert stood_s(seen_at(*CAME, gone, *other), PLACES, 0.3).tolist() == [10.0, 0.0]
     assert stood_s(seen_at(*CAME, gone), PLACES, 0.3).tolist() == [0.0, 0.0]
+
+
+def test_where_the_clock_began_anew_the_time_does_as_well() -> None:
+    again = (POST, 0.5, 1.0), (POST, 0.0, 4.0)
+    assert stood_s(seen_at(*CAME, *again), PLACES, 0.3).tolist() == [3.0, 0.0]
