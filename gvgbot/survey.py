@@ -26,6 +26,7 @@ _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks
 _NEARER = 0.75  # of the clearance in the open: a coast is seen from so near
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _BODY_M = 0.45  # from the middle of somebody to where beams end on him
+_HALF_M = 0.35  # of the widest body, all round
 _STEP_M = 0.05  # between points of a way: a cell of the grid
 _EVERY = 4  # of them, from which a robot looks
 _WALL = 100  # percent
@@ -160,7 +161,7 @@ def _at_ends(pipeline: Pipeline) -> Array:
 def _may_go(places: Array, scans: Scans, pipeline: Pipeline) -> Array:
     """Those bodies (M, 2) of some (N, 2) that have not stood for so long that they stay."""
     lasting_s = pipeline.traffic.newcomers.longest_patience
-    return np.asarray(places[stood_s(scans, places, _BODY_M) < lasting_s])
+    return np.asarray(places[stood_s(scans, places, _HALF_M) < lasting_s])
 
 
 def _barred(

@@ -71,7 +71,7 @@ class Hazards:
     def take_over(self, other: "Hazards", other_own: Pose, metres: float) -> None:
         """Go on in another's local frame, which sees this one's at a pose, with what it has felt.
 
-        Since it began to count so many metres had been driven.
+        It began to count when so many metres had been driven.
         """
         for hazard in self.felt:
             hazard.points = other_own.transform(hazard.points)

@@ -25,7 +25,8 @@ from gvgbot.autonomy.views import Correspondence, Observation, View, touches
 from gvgbot.geometry import Array, Pose
 
 _ODD = 9.0  # squared Mahalanobis distance, 2 degrees of freedom, of a sight that counts less
-_WALLS, _ROOMIER_M = 3, 0.05  # around a meetpoint or an endpoint; by which one place beats another
+_WALLS = 3  # that a meetpoint or an endpoint lies between
+_ROOMIER_M = 0.05  # by which one place beats another
 _ELSEWHERE, _IN_A_ROW = 18.0, 3  # the same of sights that show, so many, that it stands elsewhere
 _TOGETHER = 1.6  # times the sigma of each, as the sights of one visit err together
 _MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
@@ -235,8 +236,9 @@ class Mapper(MapEdits):
         r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, own)
         off = ekf.mahalanobis(r, S)
         if vertex.settled and away < self._config.trust_m:
-            is_elsewhere = off > _ELSEWHERE and not self._is_still_there(view, vertex)
-            vertex.elsewhere = vertex.elsewhere + 1 if is_elsewhere else 0
+            if off > _ELSEWHERE and self._is_still_there(view, vertex):
+                return
+            vertex.elsewhere = vertex.elsewhere + 1 if off > _ELSEWHERE else 0
         if vertex.elsewhere >= _IN_A_ROW:
             self._place_anew(view, vertex)
             return

@@ -42,21 +42,26 @@ def stood_s(scans: Scans, places: Array, within_m: float) -> Array:
     before = -np.inf
     for map_base, scan, found in _looks(scans, places, within_m):
         if scan.stamp < before:
-            first[:] = last[:] = np.nan
+            first[:] = np.nan
         before = scan.stamp
-        for place in np.flatnonzero(np.isfinite(first) & _in_view(scan, map_base, places)):
+        is_hit = np.zeros(len(places), np.bool_)
+        is_hit[found] = True
+        for place in np.flatnonzero(
+            (np.isfinite(first) | is_hit) & _in_view(scan, map_base, places)
+        ):
             if is_seen_through(scan, map_base, (places[place], _CORE_M)):
-                first[place] = last[place] = np.nan
-        first[found] = np.where(np.isnan(first[found]), scan.stamp, first[found])
-        last[found] = scan.stamp
+                first[place], is_hit[place] = np.nan, False  # it was the wall behind
+        first[is_hit & np.isnan(first)] = scan.stamp
+        last[is_hit] = scan.stamp
     return np.asarray(np.nan_to_num(last - first))
 
 
 def _in_view(scan: Scan, map_base: Pose, places: Array) -> NDArray[np.bool_]:
-    """Whether the beam towards each of the places (N, 2), map frame, gets as far as that."""
+    """Whether beams towards each of the places (N, 2), map frame, get as far as that."""
     x, y = map_base.compose(scan.base_laser).inverse().transform(places).T
     beam = np.round((np.arctan2(y, x) - scan.angle_min) % math.tau / scan.angle_increment)
-    told = scan.ranges[np.minimum(beam.astype(np.intp), len(scan.ranges) - 1)]
+    beside = np.add.outer([-1, 0, 1], beam.astype(np.intp)).clip(0, len(scan.ranges) - 1)
+    told = np.fmax.reduce(scan.ranges[beside])  # one of them may have no echo
     return np.asarray((beam < len(scan.ranges)) & (told > np.hypot(x, y)))
 
 

@@ -38,6 +38,7 @@ class RunDirectory:
         self.path = path
         try:
             path.mkdir(parents=True, exist_ok=True)
+            self._device = path.parent.stat().st_dev
             self._events = _list_of_events(path / EVENTS)
         except OSError as error:
             raise _unfit(path, error) from error
@@ -96,9 +97,10 @@ class RunDirectory:
             raise GvgbotError(f"cannot write {self.path / EVENTS}: {error.strerror}") from error
 
     def _make_again(self) -> None:
-        """Make the directory, if somebody has removed it; the one around it goes with its disk."""
+        """Make the directory, if somebody has removed it and not pulled out its disk."""
         with contextlib.suppress(OSError):  # whoever writes there tells
-            self.path.mkdir()
+            if self.path.parent.stat().st_dev == self._device:
+                self.path.mkdir()
 
     def _turn_over(self) -> None:
         """Begin a new list of events; go on with the old one if that is not possible."""

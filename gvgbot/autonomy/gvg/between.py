@@ -1,5 +1,6 @@
 """What walls a place lies between: a meetpoint is equally far from three or more."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,8 @@ from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.geometry import Array
 
 _EQUAL_M = 0.1  # walls that are so much farther off count as equally near
-_APART_RAD = 0.35  # directions to points of one wall are closer
+_APART_RAD = 0.35  # directions to points of one wall are closer,
+_APART_M = 0.1  # and so are the points
 
 
 class Between(NamedTuple):
@@ -19,7 +21,7 @@ class Between(NamedTuple):
 
 
 def between(local_map: LocalMap, place: Array) -> Between:
-    """What walls of a map a place (2,), local frame, lies between; a round one counts as two."""
+    """What walls of a map a place (2,), local frame, lies between; a round one counts as many."""
     tree = local_map.tree()
     clearance = float(tree.query(place)[0])
     near = local_map.points()[tree.query_ball_point(place, clearance + _EQUAL_M)] - place
@@ -27,8 +29,11 @@ def between(local_map: LocalMap, place: Array) -> Between:
         return Between(clearance, 0)
     bearings = np.sort(np.arctan2(near[:, 1], near[:, 0]))
     gaps = np.diff(bearings, append=bearings[0] + 2.0 * np.pi)
-    last = np.flatnonzero(gaps > _APART_RAD)  # of each wall
+    apart = max(_APART_RAD, 2.0 * math.atan2(_APART_M, clearance))
+    last = np.flatnonzero(gaps > apart)  # of each wall
     first = (np.roll(last, 1) + 1) % len(bearings)
     widths = (bearings[last] - bearings[first]) % (2.0 * np.pi)
-    flat = 2.0 * np.arccos(clearance / (clearance + _EQUAL_M))  # as wide as such a wall is seen
-    return Between(clearance, int(np.sum(1 + (widths > 2.0 * flat))) if len(last) else 3)
+    flat = 2.0 * math.acos(clearance / (clearance + _EQUAL_M))  # as wide as such a wall is seen
+    if not len(last):  # it is all around
+        widths = np.array([2.0 * np.pi])
+    return Between(clearance, int(np.sum(1 + widths // (2.0 * flat))))

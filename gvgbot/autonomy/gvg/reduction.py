@@ -25,7 +25,7 @@ from gvgbot.ranges import Range
 
 _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
 _REACH_HYSTERESIS = 1.12
-_END_REACH = 1.6  # of a niche that an edge ends in, beside corners; one in a right angle has 1.41
+_END_REACH = 1.6  # of a niche that an edge ends in, or a corner of 77 degrees; a right one has 1.41
 _SEEN_SHARE = 0.8  # of the laser's range: walls farther off may lack
 _CORNER_SHARE = 0.7  # of the map's reach: a corner is sqrt(2) times as far as its walls
 _SPECK = 4.0  # so many of the shortest edges around open space are no way round it
@@ -120,8 +120,8 @@ def _prune(draft: Draft, min_reach: float, endpoints: Array) -> None:
 def _corners(
     draft: Draft, base: int, doomed: list[tuple[int, int]], endpoints: Array
 ) -> list[tuple[int, int]]:
-    """Those of the doomed leaves of a base that go: all but a niche that its only edge ends in."""
-    if draft.degree(base) - len(doomed) > 1:
+    """Those of the doomed leaves of a base that go: not the niche that its only edge ends in."""
+    if draft.degree(base) - len(doomed) != 1:
         return doomed
     deepest = max(doomed, key=lambda leaf: draft.reach(leaf[0])[0])
     share = draft.reach(deepest[0])[0] / _END_REACH

@@ -34,7 +34,7 @@ from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn, resampled
-from tests.unit.autonomy.sights import carved, looked, sweep
+from tests.unit.autonomy.sights import Rectangle, carved, looked, sweep
 from tests.unit.autonomy.slam.beliefs import updated
 
 CONFIG = MappingConfig()
@@ -192,13 +192,23 @@ def test_a_vertex_beside_which_somebody_stood_is_placed_where_it_is_seen_later()
         np.testing.assert_allclose(ends, [start.position, end.position], atol=0.06)
 
 
-def test_a_vertex_between_the_walls_it_was_found_between_stays() -> None:
-    """Part of the floor around it has been forgotten, and the GVG of the rest passes by it."""
-    room = looked(carved([(1.8, -1.2, 4.2, 1.2)]), [Pose(3.0, 0.0)])
+@pytest.mark.parametrize(
+    ("room", "stays"),
+    [
+        ([(1.8, -1.2, 4.2, 1.2)], True),  # what is known of its floor now has its middle elsewhere
+        ([(-2.0, -1.2, 3.4, 1.2), (3.4, -0.9, 8.0, 0.9)], False),  # nothing is between two walls
+        ([(2.2, -0.8, 3.2, 0.8), (3.2, -1.2, 8.0, 1.2)], False),  # there is more room elsewhere
+    ],
+)
+def test_a_vertex_stays_between_the_walls_it_was_found_between(
+    room: list[Rectangle], stays: bool
+) -> None:
+    local_map = looked(carved(room), [Pose(3.0, 0.5), Pose(3.5, 0.0)])
     seen = Seen().look(TEE, 30)
     aside = drawn(TEE_POINTS | {2: (3.5, 0.0)}, TEE_LINES, unseen=UNSEEN)
-    seen.look(aside, 60, local_map=room)
-    assert of_type(seen.events, VertexMoved) == []
+    seen.look(aside, 400, local_map=local_map)
+    assert (of_type(seen.events, VertexMoved) == []) == stays
+    assert seen.places("meetpoint") == [pytest.approx((3.0 if stays else 3.5, 0.0), abs=0.03)]
 
 
 def test_what_lies_on_an_edge_nearer_than_its_walls_lies_on_a_way() -> None:

@@ -72,3 +72,23 @@ def test_who_stands_where_somebody_has_gone_has_not_stood_there_before() -> None
 def test_where_the_clock_began_anew_the_time_does_as_well() -> None:
     again = (POST, 0.5, 1.0), (POST, 0.0, 4.0)
     assert stood_s(seen_at(*CAME, *again), PLACES, 0.3).tolist() == [3.0, 0.0]
+
+
+def test_the_wall_behind_somebody_is_not_somebody() -> None:
+    """He stands 0.4 m before it, beside which a scan sees that he is not there."""
+    near = np.array([[2.0, 0.6]])
+    came = *((WALLED, 0.0, t) for t in (0.0, 1.0)), *((POST, 0.0, t) for t in (130.0, 132.0))
+    assert stood_s(seen_at(*came), near, 0.45).tolist() == [2.0]
+    gone = *came, (WALLED, 0.5, 300.0), (POST, 0.0, 400.0), (POST, 0.0, 401.0)
+    assert stood_s(seen_at(*gone), near, 0.45).tolist() == [1.0]
+
+
+def test_a_laser_off_the_middle_of_the_base_sees_through_as_well() -> None:
+    scans = [
+        (
+            pose.compose(Pose(-0.4, 0.3, 0.5).inverse()),
+            replace(scan.unpacked(), base_laser=Pose(-0.4, 0.3, 0.5)),
+        )
+        for pose, scan in seen_at(*CAME, (WALLED, 1.0, 60.0), (POST, 0.5, 130.0))
+    ]
+    assert stood_s(scans, PLACES, 0.3).tolist() == [0.0, 0.0]

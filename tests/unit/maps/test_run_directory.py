@@ -2,6 +2,7 @@ import errno
 import json
 import math
 import shutil
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -231,6 +232,19 @@ def test_a_directory_is_not_made_where_its_disk_has_gone(tmp_path: Path) -> None
         with pytest.raises(GvgbotError, match="No such file"):
             directory.write({"map.geojson": "{}"})
         assert names(tmp_path / "disk") == set()
+
+
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a second file system")
+def test_a_directory_is_not_made_on_the_disk_below_the_one_that_has_gone(tmp_path: Path) -> None:
+    mounted, at = tmp_path / "disk", tmp_path / "mnt"
+    mounted.mkdir()
+    at.symlink_to(mounted)
+    with tempfile.TemporaryDirectory(dir="/dev/shm") as below, RunDirectory(at / "run") as run:
+        at.unlink()
+        at.symlink_to(below)
+        with pytest.raises(GvgbotError, match="No such file"):
+            run.append_event(LoopClosed(1.0, 3, 0.5))
+        assert names(Path(below)) == set()
 
 
 def test_a_list_of_events_that_came_with_another_disk_stays(tmp_path: Path) -> None:

@@ -226,8 +226,8 @@ def test_a_recess_goes_on_beside_a_desk_where_a_robot_fits_in(with_desk: bool) -
 @pytest.mark.parametrize("with_box", [False, True])
 def test_a_box_in_its_corner_makes_a_recess_no_deeper(with_box: bool) -> None:
     """It is hardly deeper than wide: no more than a wide place of the corridor."""
-    box = (-1.18, -2.3, -0.94, -2.06)
-    rooms = [(-6.0, -0.8, 6.0, 0.8), (-1.18, -2.3, 1.18, 0.8)]
+    box = (-1.18, -2.45, -0.94, -2.21)
+    rooms = [(-6.0, -0.8, 6.0, 0.8), (-1.18, -2.45, 1.18, 0.8)]
     world = carved(rooms, [box] if with_box else [])
     gvg = seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
     assert not any(tip[1] < -0.9 for tip in endpoints(gvg))

@@ -129,6 +129,31 @@ def test_what_is_worth_a_visit_does_not_grow_with_the_space_before_it() -> None:
     assert degrees(reduce_graph(corner_of_a_hall(), CONFIG)) == []
 
 
+@pytest.mark.parametrize(
+    ("left", "right", "known", "end"),
+    [
+        (1.65, 1.45, None, 0.65),  # a niche
+        (1.55, 1.45, None, 0.0),  # two corners
+        (1.65, 1.45, ended(0.0), 0.0),  # the map has the dead end where they fork
+        (1.55, 1.45, ended(0.55), 0.55),  # or in the niche
+        (1.62, 1.66, ended(0.62), 0.62),  # or in one of two
+    ],
+)
+def test_an_edge_that_forks_into_corners_ends_in_the_one_that_is_a_niche(
+    left: float, right: float, known: KnownVertices | None, end: float
+) -> None:
+    tips = [(0.0, (left - 1) * CLEARANCE), (0.0, (1 - right) * CLEARANCE)]
+    gvg = reduce_graph(fine([((-6, 0), (0, 0)), *(((0, 0), tip) for tip in tips)]), CONFIG, known)
+    assert degrees(gvg) == []
+    (found,) = (node.position for node in gvg.nodes.values() if node.position[0] > -1.0)
+    assert found == pytest.approx([0.0, end], abs=0.01)
+
+
+def test_where_all_branches_are_corners_there_is_no_edge() -> None:
+    tips = [(0.65, 0.0), (-0.6, 0.0), (0.0, 0.6)]
+    assert not reduce_graph(fine([((0, 0), tip) for tip in tips]), CONFIG).edges
+
+
 def test_twigs_of_a_corner_branch_do_not_shift_the_dead_end() -> None:
     """A room 4 m wide and 5.2 m deep, as its middle line has it; in one corner stands something."""
     door, near, far, fork = (0.0, -6.0), (0.0, -1.2), (0.0, 0.0), (1.0, -2.2)
