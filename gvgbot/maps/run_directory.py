@@ -36,6 +36,7 @@ class RunDirectory:
         directory cannot be written to.
         """
         self.path = path
+        self.on_made_again: Callable[[], None] = lambda: None  # when it had been removed
         try:
             path.mkdir(parents=True, exist_ok=True)
             self._device = path.parent.stat().st_dev
@@ -98,9 +99,10 @@ class RunDirectory:
 
     def _make_again(self) -> None:
         """Make the directory, if somebody has removed it and not pulled out its disk."""
-        with contextlib.suppress(OSError):  # whoever writes there tells
+        with contextlib.suppress(OSError, UsageError):  # whoever writes there tells
             if self.path.parent.stat().st_dev == self._device:
                 self.path.mkdir()
+                self.on_made_again()
 
     def _turn_over(self) -> None:
         """Begin a new list of events; go on with the old one if that is not possible."""

@@ -3,9 +3,10 @@
 import fcntl
 import os
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import structlog
@@ -76,7 +77,7 @@ def begin(wanted: Wanted, *, world: str, stack: ExitStack) -> Start:
         return again
     known = None if wanted.known is None else _known(wanted.known)
     directory = stack.enter_context(_new(wanted, world))
-    stack.enter_context(held(directory.path))
+    directory.on_made_again = stack.enter_context(held(directory.path))
     return Start(directory, MissionFiles(directory.path), known)
 
 
@@ -85,7 +86,7 @@ def _resumed(wanted: Wanted, stack: ExitStack) -> Start | None:
     begun_with = None if wanted.known is None else _named(wanted.known)
     for path in _newest_first(wanted.state_dir):
         with ExitStack() as held_here:
-            held_here.enter_context(held(path))  # first: what is read may still grow otherwise
+            hold = held_here.enter_context(held(path))  # first: what is read may grow otherwise
             files = MissionFiles(path)
             try:
                 saved = files.read()
@@ -99,6 +100,7 @@ def _resumed(wanted: Wanted, stack: ExitStack) -> Start | None:
             if begun_with is not None and (saved is None or saved.known != begun_with):
                 return None
             directory = held_here.enter_context(RunDirectory(path))
+            directory.on_made_again = hold
             stack.enter_context(held_here.pop_all())
             return Start(directory, files, saved)
     return None
@@ -110,23 +112,27 @@ def _named(path: Path) -> str:
 
 
 @contextmanager
-def held(path: Path) -> Iterator[None]:
+def held(path: Path) -> Iterator[Callable[[], None]]:
     """Keep other programs from writing a run to this directory meanwhile.
 
+    What is yielded does so once more, where the directory has been removed and made again.
     Raises UsageError if one does so already. The kernel lets go of it whatever ends this program.
     """
+    with ExitStack() as holds:
+        hold = partial(_hold, path, holds)
+        hold()
+        yield hold
+
+
+def _hold(path: Path, holds: ExitStack) -> None:
     directory = os.open(path, os.O_RDONLY)
+    holds.callback(os.close, directory)
     try:
         fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
-        os.close(directory)
         raise UsageError(f"{path} is in use: another gvgbot run writes to it; stop that") from error
     except OSError as error:  # not every network file system can do this
         log.debug("run directory not held", reason=str(error))
-    try:
-        yield
-    finally:
-        os.close(directory)
 
 
 def _new(wanted: Wanted, world: str) -> RunDirectory:

@@ -189,6 +189,22 @@ def test_a_mission_is_not_read_while_another_program_writes_to_it(tmp_path: Path
         pass
 
 
+@pytest.mark.parametrize("is_resumed", [False, True])
+def test_a_directory_that_is_made_again_is_held_again(tmp_path: Path, is_resumed: bool) -> None:
+    if is_resumed:
+        mission(tmp_path / "runs" / "office-1")
+    with ExitStack() as stack:
+        start = begin(Wanted(state_dir=tmp_path), world="office", stack=stack)
+        path = start.directory.path
+        assert (start.saved is not None) == is_resumed
+        shutil.rmtree(path)
+        start.directory.write({"map.geojson": "{}"})
+        with pytest.raises(UsageError, match="in use"), held(path):
+            pass
+    with held(path):
+        pass
+
+
 def test_links_in_a_ring_are_no_map(tmp_path: Path) -> None:
     (tmp_path / "ring").symlink_to(tmp_path / "ring")
     with pytest.raises(UsageError, match="cannot begin with"):
