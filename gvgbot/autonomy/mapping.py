@@ -237,6 +237,7 @@ class Mapper(MapEdits):
         off = ekf.mahalanobis(r, S)
         if vertex.settled and away < self._config.trust_m:
             if off > _ELSEWHERE and self._is_still_there(view, vertex):
+                vertex.elsewhere = 0
                 return
             vertex.elsewhere = vertex.elsewhere + 1 if off > _ELSEWHERE else 0
         if vertex.elsewhere >= _IN_A_ROW:

@@ -26,7 +26,7 @@ Scans = Sequence[tuple[Pose, AnyScan]]  # where each was taken (map_base)
 def hits(scans: Scans, places: Array, within_m: float) -> NDArray[np.int64]:
     """How many scans hit something near places (N, 2), m, map frame; each hit is the nearest's."""
     looks = np.zeros(len(places), np.int64)
-    for _, _, found in _looks(scans, places, within_m):
+    for _, _, found in _with_hits(scans, places, within_m):
         looks[found] += 1
     return looks
 
@@ -40,7 +40,7 @@ def stood_s(scans: Scans, places: Array, within_m: float) -> Array:
     """
     first, last = np.full(len(places), np.nan), np.full(len(places), np.nan)
     before = -np.inf
-    for map_base, scan, found in _looks(scans, places, within_m):
+    for map_base, scan, found in _with_hits(scans, places, within_m):
         if scan.stamp < before:
             first[:] = np.nan
         before = scan.stamp
@@ -65,7 +65,7 @@ def _in_view(scan: Scan, map_base: Pose, places: Array) -> NDArray[np.bool_]:
     return np.asarray((beam < len(scan.ranges)) & (told > np.hypot(x, y)))
 
 
-def _looks(
+def _with_hits(
     scans: Scans, places: Array, within_m: float
 ) -> Iterator[tuple[Pose, Scan, NDArray[np.intp]]]:
     """All scans, with where they were taken and which of the places (N, 2) they hit."""

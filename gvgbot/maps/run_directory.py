@@ -86,9 +86,9 @@ class RunDirectory:
         Raises TypeError if the event is no dataclass, GvgbotError if the line cannot be written.
         """
         line = json.dumps(record_of(event), ensure_ascii=False, allow_nan=False) + "\n"
-        self._make_again()
         try:
             if not _is_at(self._events, self.path / EVENTS):
+                self._make_again()
                 before, self._events = self._events, _list_of_events(self.path / EVENTS)
                 before.close()
             _append(self._events, line.encode())

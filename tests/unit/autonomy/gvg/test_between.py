@@ -14,16 +14,8 @@ from gvgbot.worlds.canvas import Canvas
 from tests.unit.autonomy.sights import carved, looked
 
 CORRIDOR = (-6.0, -1.0, 6.0, 1.0)
-TEE = carved(
-    [CORRIDOR, (-1.0, -6.0, 1.0, 1.0)]
-)  # from (0, -0.25) both corners are as far as the wall
-ROUND = 2.0
-
-
-def disc() -> World:
-    canvas = Canvas(6.0, 6.0, 0.02)
-    canvas.carve_disc(3.0, 3.0, ROUND)
-    return replace(canvas.world("disc"), origin=(-3.0, -3.0))
+# From (0, -0.25) both corners are as far as the wall.
+TEE = carved([CORRIDOR, (-1.0, -6.0, 1.0, 1.0)])
 
 
 @pytest.mark.parametrize(
@@ -55,7 +47,10 @@ def test_it_lies_between_the_walls_that_are_equally_near(
 
 
 def test_a_round_wall_is_on_all_sides() -> None:
-    local_map = looked(disc(), [Pose(0.0, 0.0, math.pi / 4)])
+    canvas = Canvas(6.0, 6.0, 0.02)
+    canvas.carve_disc(3.0, 3.0, 2.0)
+    world = replace(canvas.world("disc"), origin=(-3.0, -3.0))
+    local_map = looked(world, [Pose(0.0, 0.0, math.pi / 4)])
     assert between(local_map, np.zeros(2)).walls >= 3
 
 

@@ -11,6 +11,7 @@ from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.sights import (
     LASER_270,
     RADIUS,
+    Rectangle,
     all_points,
     carved,
     endpoints,
@@ -194,13 +195,16 @@ def test_a_recess_much_deeper_than_the_clearance_before_it_is_a_dead_end() -> No
     assert is_near(ends[ends[:, 1] < -1.0], [(0.0, -3.4)], NOISY)
 
 
+def beside_recess(back: float, *furniture: Rectangle) -> LocalGvg:
+    """The GVG of a corridor and a recess of 2.36 m up to y = `back`, as seen from the corridor."""
+    world = carved([(-6.0, -0.8, 6.0, 0.8), (-1.18, back, 1.18, 0.8)], furniture)
+    return seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
+
+
 @pytest.mark.parametrize("with_desk", [False, True])
 def test_a_recess_is_as_deep_with_a_desk_in_its_corner(with_desk: bool) -> None:
     """Up to (0, -1.62), as far from its sides as from its back; or as from the desk before it."""
-    desk = (-1.18, -2.8, -0.38, -2.2)
-    rooms = [(-6.0, -0.8, 6.0, 0.8), (-1.18, -2.8, 1.18, 0.8)]
-    world = carved(rooms, [desk] if with_desk else [])
-    gvg = seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
+    gvg = beside_recess(-2.8, *([(-1.18, -2.8, -0.38, -2.2)] if with_desk else []))
     assert is_near(meetpoints(gvg), [(0.0, -(2.36**2) / (8 * 1.6))], NOISY)
     (end,) = (tip for tip in endpoints(gvg) if tip[1] < -0.9)
     if with_desk:
@@ -210,26 +214,18 @@ def test_a_recess_is_as_deep_with_a_desk_in_its_corner(with_desk: bool) -> None:
         assert end == pytest.approx([0.0, -2.8 + 1.18], abs=NOISY)
 
 
-@pytest.mark.parametrize("with_desk", [False, True])
-def test_a_recess_goes_on_beside_a_desk_where_a_robot_fits_in(with_desk: bool) -> None:
+def test_a_recess_goes_on_beside_a_desk_where_a_robot_fits_in() -> None:
     """Its end is as far from the desk's side as from its own side and back."""
-    desk = (-1.18, -3.16, -0.38, -2.36)
-    rooms = [(-6.0, -0.8, 6.0, 0.8), (-1.18, -3.16, 1.18, 0.8)]
-    world = carved(rooms, [desk] if with_desk else [])
-    gvg = seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
-    left, right, back = -0.38 if with_desk else -1.18, 1.18, -3.16
+    gvg = beside_recess(-3.16, (-1.18, -3.16, -0.38, -2.36))
     (end,) = (tip for tip in endpoints(gvg) if tip[1] < -0.9)
-    middle, half = (left + right) / 2, (right - left) / 2
-    assert end == pytest.approx([middle, back + half], abs=NOISY)
+    middle, half = (-0.38 + 1.18) / 2, (1.18 - -0.38) / 2
+    assert end == pytest.approx([middle, -3.16 + half], abs=NOISY)
 
 
 @pytest.mark.parametrize("with_box", [False, True])
 def test_a_box_in_its_corner_makes_a_recess_no_deeper(with_box: bool) -> None:
     """It is hardly deeper than wide: no more than a wide place of the corridor."""
-    box = (-1.18, -2.45, -0.94, -2.21)
-    rooms = [(-6.0, -0.8, 6.0, 0.8), (-1.18, -2.45, 1.18, 0.8)]
-    world = carved(rooms, [box] if with_box else [])
-    gvg = seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
+    gvg = beside_recess(-2.45, *([(-1.18, -2.45, -0.94, -2.21)] if with_box else []))
     assert not any(tip[1] < -0.9 for tip in endpoints(gvg))
     assert len(meetpoints(gvg)) == 0
 
